@@ -19,6 +19,7 @@ from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.ikurt.metric import TipMetric
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
+from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.world.problem import Problem
 
 WRIST = "titan4_wrist"
@@ -31,6 +32,8 @@ RULES = {
     "samples beyond the limits": replace(LETTER, beyond=BEYOND),
     "directions of equal chance": replace(LETTER, even=True),
 }
+ANYWHERE = (SLOW_RULE, "samples beyond the limits", "directions of equal chance")  # compared at random poses
+RANDOM_POSES, RANDOM_EVALUATIONS = 12, 15_000
 EVALUATIONS, FEW_EVALUATIONS = 20_000, 5_000  # of the metric, after which a run ends
 BUDGET = "evaluations of the metric; step, threshold and accuracy are chosen here: none is printed"
 
@@ -124,6 +127,54 @@ def limits(quick: bool) -> list[Row]:
     return rows
 
 
+def random_poses(quick: bool) -> list[Row]:
+    """Poses of random postures of TITAN-4 without obstacles, by the letter and with one change at a time."""
+    count, most = (3, FEW_EVALUATIONS) if quick else (RANDOM_POSES, RANDOM_EVALUATIONS)
+    problems = [_random_problem(seed) for seed in range(count)]
+    rooms = np.array([_room(problem) for problem in problems])
+    rows = []
+    arrived = {}
+    for rule in ANYWHERE:
+        searches = [letter_search(problem, RULES[rule], 0, most) for problem in problems]
+        arrived[rule] = np.array([search.run() is not None for search, _ in searches])
+        nearest = np.array([watched.nearest[-1] for _, watched in searches]) / METRIC
+        text = (
+            f"{arrived[rule].sum()} of {count}; the others end at {_span(nearest[~arrived[rule]])} times the accuracy"
+        )
+        label, reading = f"random poses: {rule}", f"at most {most} {BUDGET}"
+        if rule == SLOW_RULE:
+            rows.append(Row(label, PRINTED[rule], text, None, f"{reading}; not only goals at limits are slow"))
+        else:
+            more = float(arrived[rule].sum() - arrived[SLOW_RULE].sum()) / count
+            rows.append(judged(label, "not in the print", text, more, Bar((-1.0, 1.0), held=(1e-9, 1.0)), reading))
+
+    slow = ~arrived[SLOW_RULE]
+    text = f"arrived: {_span(rooms[~slow])} deg; not: {_span(rooms[slow])} deg"
+    reading = "of the nearest joint from its limit, at the solution that has the most room"
+    rows.append(Row("random poses: room to the limits", "not in the print", text, None, reading))
+    return rows
+
+
+def _random_problem(seed: int) -> Problem:
+    """The pose of a random posture, from the start of the regular example."""
+    example = rrtik.load_problem("titan4_regular")
+    robot = example.robot
+    q = np.random.default_rng([5, seed]).uniform(robot.lower, robot.upper)
+    return as_published(Problem(example.world, example.start, PoseGoal(robot.fk(q))))
+
+
+def _room(problem: Problem) -> float:
+    """How far the nearest joint is from its limit [deg], at the solution of a pose where that is most."""
+    robot = problem.robot
+    Q = rrtik.solve_ik(robot, problem.goal, method="closed-form", all=True).solutions  # type: ignore[arg-type]
+    return float(np.degrees(np.minimum(Q - robot.lower, robot.upper - Q).min(axis=1).max()))
+
+
+def _span(values: Vector) -> str:
+    """Median, and from least to most; "none" if there are no values."""
+    return f"{np.median(values):.2g} ({values.min():.2g} to {values.max():.2g})" if len(values) else "none"
+
+
 PRINTED = {"to the letter": "solved; no time", "blocked steps tolerated": "no help, if none is blocked"}
 BARS = {
     "blocked steps tolerated": Bar((0.0, 1.0), held=(0.0, 0.4)),
@@ -140,5 +191,14 @@ TABLES = (
         80,
         6,
         bars="the source says that they are solved; evaluations and shares ours",
+    ),
+    Table(
+        "ikurt-random",
+        "Random poses: one change at a time",
+        SOURCE,
+        random_poses,
+        150,
+        12,
+        bars="the source says that poses are solved; evaluations and shares ours",
     ),
 )

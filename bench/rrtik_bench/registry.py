@@ -15,6 +15,7 @@ from rrtik_bench import (
     titan4_screws,
     titan4_tracking,
 )
+from rrtik_bench.crdt import passages
 from rrtik_bench.crdt import tables as crdt
 from rrtik_bench.errata import tables as errata
 from rrtik_bench.figures import crdt as crdt_figures
@@ -35,7 +36,19 @@ from rrtik_bench.shortening import tables as shortening
 from rrtik_bench.tables import Collection
 
 PAGES = (
-    *(titan4, titan4_screws, titan4_tracking, mb_rrt, mb_rrt_beyond, genetic, coding, crdt, ikurt, ikurt_limits),
+    *(
+        titan4,
+        titan4_screws,
+        titan4_tracking,
+        mb_rrt,
+        mb_rrt_beyond,
+        genetic,
+        coding,
+        crdt,
+        passages,
+        ikurt,
+        ikurt_limits,
+    ),
     *(drrt_con, drrt_con_scenes, reshaping, in_time, shortening),
     *(sensing, camera_tables, sequences, detections, errata),
 )

@@ -40,6 +40,7 @@ def test_the_beginning_of_names_chooses_all_tables_of_a_page():
     assert [table.name for table in chosen(TABLES, ["sensing", "mb-rrt-8"])] == [
         "mb-rrt-8",
         "sensing-arithmetic",
+        "sensing-shape",
         "sensing-noise",
         "sensing-precision",
         "sensing-gripper",

@@ -9,7 +9,7 @@ import numpy as np
 from rrtik_bench.report.figures import Figure
 from rrtik_bench.sensing.detections import NUMBERS, confusion
 from rrtik_bench.sensing.sequences import APART, NEAR, errors
-from rrtik_bench.sensing.tables import ACCURACY, SERIES, simulated
+from rrtik_bench.sensing.tables import ACCURACY, COORDINATES, simulated
 from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
@@ -17,12 +17,15 @@ if TYPE_CHECKING:
 
 
 def precision(drawing: Drawing, quick: bool) -> None:
-    """Standard deviation of the depth by distance, simulated and printed."""
+    """Standard deviations of a marker's place by its distance, simulated and printed."""
     panel = drawing.subplots()
-    distance, printed = (np.array([row[k] for row in SERIES]) for k in (2, 3))
-    panel.plot(distance, [row.value for row in simulated(quick)], "o-", color=COLORS[0], label="simulated, 0.03 px")
-    panel.plot(distance, printed, "x", color=COLORS[1], markersize=10, label="published")
-    panel.set(xlabel="distance [mm]", ylabel="standard deviation of z [mm]", yscale="log")
+    distance = [series[2][2] for series in COORDINATES]
+    ours = np.array([row.value for row in simulated(quick)]).reshape(-1, 3)
+    for k, axis in enumerate("xyz"):
+        printed = [series[k][3] for series in COORDINATES]
+        panel.plot(distance, ours[:, k], "-", color=COLORS[k], label=f"{axis}, simulated, 0.03 px")
+        panel.plot(distance, printed, "x", color=COLORS[k], markersize=8, label=f"{axis}, published")
+    panel.set(xlabel="distance [mm]", ylabel="standard deviation [mm]", yscale="log")
     panel.legend(frameon=False)
     tidy(panel)
 

@@ -14,7 +14,8 @@ WORDS = frozenset({
     "end CONNECT", "far from optimal", "faster", "fewer, in words", "future work", "implied", "in the sixth frame",
     "joints may slide; none measured", "kinds are named, not counted", "named", "near the shortest",
     "no evidence that it helps", "no help, if none is blocked", "no more", "none, by implication", "not in the print",
-    "not measured", "not optimal", "not treated", "one is shown", "shorter", "smooth", "solved; no time", "usable",
+    "not measured", "not optimal", "not treated", "one is shown", "shorter", "smooth", "solved; no time",
+    "stalls, unless along the axes", "usable",
     "visible",
 })  # fmt: skip
 """What leaves the number that judges to us, or is not printed at all."""

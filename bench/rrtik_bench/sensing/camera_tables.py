@@ -11,7 +11,7 @@ import numpy as np
 
 from rrtik_bench.report.rows import Bar, Row, about, judged, within
 from rrtik_bench.sensing.precision import series_of
-from rrtik_bench.sensing.tables import ACCURACY, GRIPPER, SERIES, SOURCE
+from rrtik_bench.sensing.tables import ACCURACY, COORDINATES, GRIPPER, SOURCE
 from rrtik_bench.tables import Table
 
 TIMES_STEADIER = 3.0  # wanted of the depth of a marker; of a gripper only that it is not less steady
@@ -25,7 +25,7 @@ def precision(quick: bool) -> list[Row]:
     from rrtik_bench.sensing.runs import PLAIN, positions, random_poses, seen_poses
 
     poses, count, rows = (2, 20, []) if quick else (8, 100, [])
-    for number, (_, _, z, printed) in enumerate(SERIES, start=1):
+    for number, (_, _, (_, _, z, printed)) in enumerate(COORDINATES, start=1):
         worst = {}
         for align in (False, True):
             seen = [seen_poses([T], count, number, align=align, **PLAIN) for T in random_poses(1e-3 * z, poses, 0)]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from rrtik_bench.report.rows import Bar, Row, about, judged, within
-from rrtik_bench.sensing.precision import Series
+from rrtik_bench.report.rows import INFINITE, Bar, Row, about, judged, within
+from rrtik_bench.sensing.precision import NORMAL_QUARTILES, Series
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix, Vector
 
 SOURCE = "[1, ch. 4]"
 COUNT = 100  # observations of a series
+SAMPLES = 20_000  # normal ones, which tell what is rare
 CAMERA = np.array([[877.6915, 0.2272, 320.6451], [0.0, 869.8953, 242.8119], [0.0, 0.0, 1.0]])  # [px]
 MARKER = 80.0  # [mm]
 NOISE = 0.03  # [px] of each corner coordinate
@@ -46,8 +47,6 @@ GRIPPER = {
     1500: Series(COUNT, 2407.2225, 2398.0351, 2402.7820, 5.3397, (2400.3763, 2403.4463, 2404.6499)),
     2000: Series(COUNT, 2791.8982, 2777.4443, 2784.6694, 5.5185, (2782.7907, 2784.4271, 2787.0907)),
 }
-# Marker before the camera: mean x, y, z and standard deviation of z, per series [mm]
-SERIES = tuple((x[2], y[2], z[2], z[3]) for x, y, z in COORDINATES)
 # Two markers 300 mm apart: distance to the camera, mean and standard deviation of what was measured [mm], error [%]
 ACCURACY = (
     (600, 299.1255, 0.0432, -0.2915),
@@ -61,7 +60,7 @@ def arithmetic(quick: bool) -> list[Row]:
     """Figures that follow from others in the tables."""
     del quick
     rows = []
-    for number, printed, spread in ((1, 0.0067, SERIES[0][3]), (6, 0.2114, SERIES[5][3])):
+    for number, printed, spread in ((1, 0.0067, COORDINATES[0][2][3]), (6, 0.2114, COORDINATES[5][2][3])):
         ours = spread / np.sqrt(COUNT)
         rows.append(judged(f"test 1, series {number}: precision of the mean", f"{printed} mm", f"{ours:.4f} mm", ours,
                            Bar((0.0, 10.0), held=about(printed, 1e-4))))  # fmt: skip
@@ -97,27 +96,76 @@ def deviations() -> list[Row]:
 
 
 def simulated(quick: bool) -> list[Row]:
-    """The standard deviation of z that a camera with noise of 0.03 px at the corners has."""
+    """The standard deviations that a camera with noise of 0.03 px at the corners has; the noise was fitted to z."""
     del quick
     rows = []
-    for number, (x, y, z, printed) in enumerate(SERIES, start=1):
-        ours = _spread_of_z(np.array([x, y, z]))
-        rows.append(
-            judged(f"series {number}, z = {z:.0f} mm: standard deviation of z", f"{printed} mm", f"{ours:.3f} mm", ours,
-                   Bar((0.0, 100.0), held=within(1.5, printed), differs=within(2.0, printed) if z > FAR else None),
-                   "propagated to first order, marker parallel to the picture")
-        )  # fmt: skip
+    for number, series in enumerate(COORDINATES, start=1):
+        place = np.array([mean for _, _, mean, _ in series])
+        z = place[2]
+        for axis, (_, _, _, printed), ours in zip("xyz", series, _spreads(place), strict=True):
+            bar = Bar((0.0, 100.0), held=within(1.5, printed), differs=within(2.0, printed) if z > FAR else None)
+            reading = "propagated to first order, marker parallel to the picture"
+            if axis != "z":
+                bar = Bar((0.0, 100.0), held=within(1.5, printed), differs=within(3.0, printed))
+                reading += "; by the noise fitted to z, if corners err independently: common errors shift x and y alone"
+            name = f"series {number}, z = {z:.0f} mm: standard deviation of {axis}"
+            digits = 3 if axis == "z" else 4
+            rows.append(judged(name, f"{printed} mm", f"{ours:.{digits}f} mm", ours, bar, reading))
     return rows
 
 
-def _spread_of_z(place: Vector) -> float:
-    """By the Gauss-Newton covariance of a pose from its four corners [mm]."""
+def _spreads(place: Vector) -> Vector:
+    """By the Gauss-Newton covariance of a pose from its four corners [mm], shape (3,)."""
     here = np.concatenate([np.zeros(3), place])
     moves = STEP * np.diag([1.0, 1.0, 1.0, *np.full(3, place[2])])
     columns = [(_corners(here + move) - _corners(here - move)) / (2.0 * move.max()) for move in moves]
     jacobian = np.stack([column.ravel() for column in columns], axis=1)
     covariance = NOISE**2 * np.linalg.inv(jacobian.T @ jacobian)
-    return float(np.sqrt(covariance[5, 5]))
+    spreads: Vector = np.sqrt(np.diag(covariance))[3:]
+    return spreads
+
+
+def shapes(quick: bool) -> list[Row]:
+    """Whether printed extremes and quartiles are those of normal samples of 100, by 20,000 of them."""
+    del quick
+    samples = np.random.default_rng(0).normal(size=(SAMPLES, COUNT))
+    deviation = samples.std(axis=1, ddof=1)
+    low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75], axis=1)
+    chance = {
+        "range": np.ptp(samples, axis=1) / deviation,
+        "quartiles": (high - low) / NORMAL_QUARTILES / deviation,
+        "median": (middle - samples.mean(axis=1)) / deviation,
+    }
+    rare = {what: _without_rare(values) for what, values in chance.items()}
+
+    rows = []
+    for number, (series, quartiles) in enumerate(zip(COORDINATES, QUARTILES, strict=True), start=1):
+        for axis, (largest, smallest, _, spread) in zip("xyz", series, strict=True):
+            rows.append(_shape(f"series {number}, {axis}: range", f"{largest:g} to {smallest:g} mm",
+                               (largest - smallest) / spread, rare["range"]))  # fmt: skip
+        _, _, mean, spread = series[2]
+        first, median, third = quartiles
+        rows.append(_shape(f"series {number}, z: between the quartiles", f"{first:g} to {third:g} mm",
+                           (third - first) / NORMAL_QUARTILES / spread, rare["quartiles"]))  # fmt: skip
+        rows.append(_shape(f"series {number}, z: median less mean", f"{median:g} mm",
+                           (median - mean) / spread, rare["median"]))  # fmt: skip
+    return rows
+
+
+def _without_rare(values: Vector) -> tuple[float, float]:
+    """What all but one in a thousand values lie between."""
+    low, high = np.quantile(values, [0.0005, 0.9995])
+    return float(low), float(high)
+
+
+def _shape(name: str, printed: str, ours: float, usual: tuple[float, float]) -> Row:
+    """A printed statistic in standard deviations; outside what is usual the sample is not normal."""
+    low, high = usual
+    text = f"{ours:.2f} of the deviation; a normal sample has {low:.2f} to {high:.2f}"
+    bar = Bar((-INFINITE, INFINITE), held=usual, differs=(low - 0.2, high + 0.2))
+    return judged(
+        name, printed, text, ours, bar, "" if low <= ours <= high else "rarer than one in a thousand normal samples"
+    )
 
 
 def _corners(pose: Vector) -> Matrix:
@@ -130,6 +178,8 @@ def _corners(pose: Vector) -> Matrix:
 
 TABLES = (
     Table("sensing-arithmetic", "Precision and accuracy: what follows", SOURCE, arithmetic, 1, 1),
+    Table("sensing-shape", "Extremes and quartiles beside normal samples", SOURCE, shapes, 1, 1,
+          bars="the source claims no distribution; what is rare, one in a thousand, is ours"),
     Table("sensing-noise", "Precision against distance, simulated", SOURCE, simulated, 1, 1,
           fitted=f"the noise of a corner, {NOISE} px"),
 )  # fmt: skip

@@ -132,6 +132,14 @@ def test_secondary_tasks_use_what_the_tip_leaves_free(panda):
         assert better(here) > better(q)
 
 
+def test_the_tip_drifts_with_the_square_of_a_step_of_secondary_tasks(panda):
+    q = panda.posture("default") + np.array([0.6, 0.3, -0.5, 0.2, 0.4, 0.0, 0.3])
+    rates = Servo(World(panda), centring=0.3).step(q, np.zeros(6), 1e-3)
+    assert np.linalg.norm(rates) > 0.05
+    drifts = [np.linalg.norm(tip(panda, q + h * rates) - tip(panda, q)) for h in (0.1, 0.05)]
+    assert drifts[0] / drifts[1] == pytest.approx(4.0, rel=0.15)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [

@@ -56,6 +56,15 @@ def test_the_tip_comes_to_the_target_within_its_speed(method):
     assert (np.abs(np.diff(rows, axis=0)) <= ROBOT.velocity * DT + 1e-12).all()
 
 
+def test_by_position_the_tip_moves_straight_and_nearer_by_the_same_share_in_each_step():
+    goal = ROBOT.fk(START) * pose_from_rpy([0.01, -0.02, 0.015], [0.0, 0.0, 0.0])
+    rows, _ = led(leading(gain=2.0, speed=1.0), lambda _: goal, 1.0)
+    from_goal = ROBOT.fk_batch(rows)[:, :3, 3] - goal.translation
+    far = np.linalg.norm(from_goal, axis=1)
+    assert far[1:] / far[:-1] == pytest.approx(1.0 - 2.0 * DT, abs=2e-3)
+    assert np.linalg.norm(np.cross(from_goal, from_goal[0] / far[0]), axis=1).max() < 0.01 * far[0]
+
+
 def test_a_swaying_target_is_followed():
     goal = ROBOT.fk(START) * pose_from_rpy([0.0, 0.0, 0.03], [0.0, 0.0, 0.1])
 
