@@ -166,7 +166,7 @@ def _random_problem(seed: int) -> Problem:
 def _room(problem: Problem) -> float:
     """How far the nearest joint is from its limit [deg], at the solution of a pose where that is most."""
     robot = problem.robot
-    Q = rrtik.solve_ik(robot, problem.goal, method="closed-form", all=True).solutions  # type: ignore[arg-type]
+    Q = rrtik.solve_ik(robot, problem.goal, method="closed-form", all=True).solutions
     return float(np.degrees(np.minimum(Q - robot.lower, robot.upper - Q).min(axis=1).max()))
 
 
