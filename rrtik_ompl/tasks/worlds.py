@@ -1,9 +1,9 @@
 """The worlds of a task, with what another instance of it has left: tables are taken over, not made again.
 
 A task needs ten worlds or more: the hand is open or closed, things stand, are held, and touch each other. From one
-instance of a task to the next most of them are the same, and in the others some obstacles stand elsewhere, which
-:meth:`rrtik_ompl.World.moved` does in place. What a world has proven before is forgotten, so that answers do not depend
-on it.
+instance of a task to the next most of them are the same. In the others some things stand elsewhere, or are held
+elsewhere, which :meth:`rrtik_ompl.World.moved` and :func:`~rrtik_ompl.world.world.held_elsewhere` do in place. What a
+world has proven before is forgotten, so that answers do not depend on it.
 """
 
 from __future__ import annotations
@@ -16,20 +16,22 @@ from dataclasses import dataclass, field
 from rrtik_ompl.base.copies import changed
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, Touching
-from rrtik_ompl.world.world import World, form_of
+from rrtik_ompl.world.world import World, form_of, held_elsewhere
 
 MOST_KEPT = 64  # worlds without contacts that are left to the next task
-MOST_MOVED = 4  # obstacles that are moved in a world; if there are more, it is made anew
+MOST_HELD = 4  # ways to hold things for each of which worlds are left; another one takes the place of the oldest
+MOST_MOVED = 4  # things that are moved in a world; if there are more, it is made anew
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Known:
     """A world without contacts, and the worlds of the same scene with contacts, by these.
 
-    The kind is what is equal for worlds that differ in the poses of obstacles alone.
+    The kind is what is equal for worlds that differ in poses alone; places are these poses, obstacles first.
     """
 
     kind: Hashable
+    places: tuple[bytes, ...]
     world: World
     in_contact: dict[tuple[Touching, ...], World] = field(default_factory=dict)
 
@@ -55,7 +57,8 @@ class Worlds:
         self._made: dict[Hashable, Known] = {}
         if not first.scene.contacts and (not self._left or _used(first)):
             kind = _kind(first.robot, first.scene)
-            self._made[kind, _places(first.scene)] = Known(kind, first)
+            places = _places(first.scene)
+            self._made[kind, places] = Known(kind, places, first)
 
     def of(self, robot: Robot, scene: Scene) -> World:
         """Return the world of a robot in a scene."""
@@ -73,7 +76,8 @@ class Worlds:
             bare = changed(scene, contacts=())
             known = self._taken_over(kind, places, bare)
             if known is None:
-                known = Known(kind, form_of(self._first, robot=robot, scene=scene if not scene.contacts else bare))
+                made = form_of(self._first, robot=robot, scene=scene if not scene.contacts else bare)
+                known = Known(kind, places, made)
             self._made[kind, places] = known
         return self._made[kind, places]
 
@@ -82,22 +86,29 @@ class Worlds:
         return [*self._left, *(known for known in self._made.values() if known.world is not self._first)]
 
     def _taken_over(self, kind: Hashable, places: tuple[bytes, ...], scene: Scene) -> Known | None:
-        """Return a world that an earlier task has left, with obstacles where they are now; None if there is none."""
+        """Return a world that an earlier task has left, with all things where they are now; None if there is none."""
         alike = [known for known in self._left if known.kind == kind]
-        if not alike:
+        standing = len(scene.obstacles)
+        held_alike = [known for known in alike if known.places[standing:] == places[standing:]]
+        same = [known for known in held_alike if known.places == places]
+        oldest = alike[:1] if len(alike) >= MOST_HELD else []
+        found = same or held_alike or oldest
+        if not found:
             return None
-        same = [known for known in alike if _places(known.world.scene) == places]
-        known = (same or alike)[-1]
+        known = found[-1]
         self._left.remove(known)
 
-        both = zip(scene.obstacles, known.world.scene.obstacles, strict=True)
-        moved = [new for new, old in both if _pose(new) != _pose(old)]
+        both = zip(_things(scene), places, known.places, strict=True)
+        moved = [thing for thing, new, old in both if new != old]
         if len(moved) > MOST_MOVED:
             return None
         world = known.world
-        for obstacle in moved:
-            world = world.moved(obstacle.name, obstacle.pose)
-        return Known(kind, world) if moved else known
+        for thing in moved:
+            if isinstance(thing, AttachedObject):
+                world = held_elsewhere(world, thing)
+            else:
+                world = world.moved(thing.name, thing.pose)
+        return Known(kind, places, world) if moved else known
 
 
 class Left(threading.local):
@@ -121,17 +132,20 @@ def _used(world: World) -> bool:
 
 
 def _kind(robot: Robot, scene: Scene) -> Hashable:
-    """Return what is equal for scenes that differ in the poses of obstacles alone."""
+    """Return what is equal for scenes that differ in poses alone."""
     obstacles = tuple((each.name, id(each.shape), each.margin, id(each.motion)) for each in scene.obstacles)
     held = tuple(
-        (each.name, each.link, id(each.shape), _pose(each), each.allow, each.padding, each.margin)
-        for each in scene.attached
+        (each.name, each.link, id(each.shape), each.allow, each.padding, each.margin) for each in scene.attached
     )
     return id(robot), obstacles, held, scene.allowed_collisions
 
 
 def _places(scene: Scene) -> tuple[bytes, ...]:
-    return tuple(map(_pose, scene.obstacles))
+    return tuple(map(_pose, _things(scene)))
+
+
+def _things(scene: Scene) -> list[Obstacle | AttachedObject]:
+    return [*scene.obstacles, *scene.attached]
 
 
 def _pose(thing: Obstacle | AttachedObject) -> bytes:

@@ -91,7 +91,7 @@ class ArmCache:
             return None
 
         table = packed.for_thread(placing=True)
-        rows = MovedSolids(table, self._robot.chain, strokes(self._robot))
+        rows = MovedSolids(table)
         return table if all(rows.put(k, bodies[k]) for k in others) else None
 
     def keep_proof(self, bodies: Sequence[Body], pairs: Pairs, packed: ProofPairs) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.base.copies import Items, Once
+from rrtik_ompl.base.copies import Items, Once, changed
 from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.geometry.collision.bodies import (
     DISTANCE_TOLERANCE,
@@ -17,6 +17,7 @@ from rrtik_ompl.geometry.collision.bodies import (
     colliding_pairs,
     far_apart,
     link_bodies,
+    mounted,
     pieces_of,
     scene_bodies,
 )
@@ -126,6 +127,31 @@ class Arrangement:
             other = replace(other, covers=covers, doubts=list(_doubts_of(obstacle)))
         return other, tuple(numbers)
 
+    def held_elsewhere(self, item: AttachedObject) -> tuple[Arrangement, tuple[int, ...]]:
+        """Return the arrangement with an attached object elsewhere on its link, and the indices of its bodies.
+
+        Args:
+            item: As it is held now: of the scene's object of its name all but the pose. The scene has no contacts.
+        """
+        _, mount = mounted(self.robot, item)
+        bodies = self.bodies
+        numbers = tuple([k for k, body in enumerate(bodies) if body.kind == "attached" and body.name == item.name])
+        for number in numbers:
+            bodies = bodies.with_(number, replace(bodies[number], placement=mount * bodies[number].within))
+
+        attached = tuple([item if each.name == item.name else each for each in self.scene.attached])
+        pairs_at_rest = self.numbers().standing(None if self.always_colliding else numbers)
+        other = replace(
+            self,
+            scene=changed(self.scene, attached=attached),
+            bodies=bodies,
+            arrays=Once(body_arrays, bodies),
+            weights=_weights(self.robot, bodies),
+            approaches=Once(_approaches, self.robot, bodies, self.checked),
+            always_colliding=_touching(bodies, pairs_at_rest),
+        )
+        return other, numbers
+
     def index_of(self, name: str) -> int:
         """Return the index of an obstacle in the scene.
 
@@ -179,7 +205,7 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
         checked=moving,
         in_contact=(),
         standing=standing,
-        weights=displacement_weights(robot, [body for body in bodies if body.kind != "obstacle"]),
+        weights=_weights(robot, bodies),
         always_colliding=fixed_contact(bodies.as_tuple, standing) is not None,
         self_margin=self_margin,
         covers=Once(arm_cache(robot).covers_of, bodies),
@@ -258,6 +284,10 @@ class Numbers:
         if moved is None:
             return tuple(dict.fromkeys(pair for pairs in self.fixed.values() for pair in pairs))
         return tuple(pair for k in moved for pair in self.fixed.get(k, ()))
+
+
+def _weights(robot: Robot, bodies: Sequence[Body]) -> Vector:
+    return displacement_weights(robot, [body for body in bodies if body.kind != "obstacle"])
 
 
 def _approaches(robot: Robot, bodies: Items[Body], pairs: Pairs) -> dict[tuple[int, int], Vector]:

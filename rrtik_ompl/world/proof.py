@@ -95,7 +95,11 @@ class Prover:
         """
         # Tables that are shared with those without contacts are not changed.
         tables = self.tables.take(numbers) if self.bare is None else TakenProof()
-        return replace(self, bodies=bodies, always_colliding=always_colliding, tables=tables, kin=object(), bare=None)
+        # Coal compares links and what they hold, wherever obstacles are.
+        coal = self._coal if all(bodies[k].kind == "obstacle" for k in numbers) else None
+        return replace(
+            self, bodies=bodies, always_colliding=always_colliding, tables=tables, kin=object(), bare=None, _coal=coal
+        )
 
     @property
     def digest(self) -> str:

@@ -129,17 +129,30 @@ class RowChecks:
             scene = exchanged(settings.scene, self.solids.index_of(obstacle.name), obstacle)
             return checks_of(changed(settings, scene=scene))
 
-        # The shared parts are held weakly, so these variables keep them alive until checks_of has found them.
-        made, numbers = derived
-        solids = ARRANGEMENTS.keep(made, settings.robot, made.scene, settings.self_margin)
-        unheld_prover = PROVERS.of(self.solids, None)
-        prover = unheld_prover.exchanged(solids.bodies, numbers, always_colliding=solids.always_colliding)
-        PROVERS.keep(prover, solids, None)
-        checks = checks_of(changed(settings, scene=solids.scene))
+        solids, numbers = derived
+        checks = self._derived(solids, numbers)
         checker = self.checker.exchanged(solids, numbers) if "checker" in vars(self) else None
         if checker is not None:
             vars(checks)["checker"] = CHECKERS.keep(checker, solids, checker.clearance)
         return checks
+
+    def held_elsewhere(self, item: AttachedObject) -> RowChecks:
+        """Return the checks with an attached object elsewhere on its link; its proofs take over the tables of these.
+
+        Args:
+            item: As it is held now: of the scene's object of its name all but the pose. The scene has no contacts.
+        """
+        return self._derived(*self.solids.held_elsewhere(item))
+
+    def _derived(self, made: Arrangement, numbers: tuple[int, ...]) -> RowChecks:
+        """Return the checks for an arrangement that differs from this one's in bodies of these indices."""
+        # The shared parts are held weakly, so these variables keep them alive until checks_of has found them.
+        settings = self.settings
+        solids = ARRANGEMENTS.keep(made, settings.robot, made.scene, settings.self_margin)
+        unheld_prover = PROVERS.of(self.solids, None)
+        prover = unheld_prover.exchanged(solids.bodies, numbers, always_colliding=solids.always_colliding)
+        PROVERS.keep(prover, solids, None)
+        return checks_of(changed(settings, scene=solids.scene))
 
     @cached_property
     def certificate(self) -> Certificate:

@@ -36,7 +36,7 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.judgement import Contact, Judge, Judged, Violation
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.world_settings import MOTION_RESOLUTION, WorldSettings, checked_settings
 from rrtik_ompl.world.certificates import Certifiable, certificate_for, fault_of
 from rrtik_ompl.world.judgement import judged_path
@@ -621,6 +621,16 @@ def form_of(world: World, **known: Any) -> World:
 def _world_of(settings: WorldSettings) -> World:
     """Create a world from valid settings: ``World(...)`` without its checks."""
     return _world_with(checks_of(settings))
+
+
+def held_elsewhere(world: World, item: AttachedObject) -> World:
+    """Return the world with an attached object elsewhere on its link, which takes over tables as :meth:`World.moved`.
+
+    Args:
+        world: The world, without contacts.
+        item: As it is held now: of the scene's object of its name all but the pose.
+    """
+    return _world_with(world.checks.held_elsewhere(item))
 
 
 def _world_with(checks: RowChecks) -> World:

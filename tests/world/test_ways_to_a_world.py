@@ -24,6 +24,7 @@ from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.world import proof
 from rrtik_ompl.world.arm_cache import ArmCache, arm_cache
+from rrtik_ompl.world.world import held_elsewhere
 from rrtik_tests.sizes import how_many
 
 UR5 = rrtik.load_robot("ur5")
@@ -311,9 +312,54 @@ def test_threads_that_remake_worlds_with_what_is_held_are_told_what_fresh_worlds
         np.testing.assert_array_equal(answer, told(seed, name))
 
 
+@pytest.mark.parametrize("name", HELD)
+def test_a_world_whose_arm_holds_a_thing_elsewhere_is_as_one_made_anew(name):
+    world = holding(SHAPES[name], 0)
+    asked(world)
+    before = world
+    for seed in range(1, 4):
+        (item,) = holding(SHAPES[name], seed).scene.attached
+        world = held_elsewhere(world, replace(item, shape=SHAPES[name]))
+        assert alike(asked(world), asked(from_nothing(world)))
+        post = thing(SHAPES["cloud"], seed)
+        world = world.moved("thing", post.pose)
+        assert alike(asked(world), asked(from_nothing(world)))
+    assert alike(asked(before), asked(from_nothing(before)))
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", HELD)
+def test_the_table_that_another_hold_takes_over_is_the_one_that_packing_makes(name, monkeypatch):
+    world = holding(SHAPES[name], 0)
+    table_of(world)
+    for seed in range(1, 4):
+        (item,) = holding(SHAPES[name], seed).scene.attached
+        taken = world.prover.tables.packed
+        world = held_elsewhere(world, item)
+        put = table_of(world)
+        assert world.prover.tables.packed is taken or name not in PUT
+        monkeypatch.setattr(ArmCache, "proof_table", lambda *_: None)
+        made = table_of(from_nothing(world))
+        monkeypatch.undo()
+        for field in put:
+            np.testing.assert_array_equal(put[field], made[field], err_msg=field)
+
+
+@pytest.mark.kernels
+def test_what_coal_has_measured_of_a_thing_is_not_said_of_it_where_it_is_held_elsewhere():
+    world = holding(SHAPES["hull"], 0)
+    measures = world.prover._coal_proof(world.prover.packed())
+    (item,) = holding(SHAPES["hull"], 1).scene.attached
+    world = held_elsewhere(world, item)
+    assert world.prover._coal_proof(world.prover.packed()) is not measures
+
+
+PUT = ("box", "ball", "cylinder", "capsule", "hull")  # put into tables where they are others
+
+
 def forbidden_for(name):
     """What packs a table, for shapes that are packed anew where they are others; nothing for all others."""
-    return None if name in ("box", "ball", "cylinder", "capsule", "hull") else proof.proof_pairs
+    return None if name in PUT else proof.proof_pairs
 
 
 @pytest.mark.kernels

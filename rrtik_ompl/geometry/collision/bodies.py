@@ -123,13 +123,12 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
                 known_names = (*links, *scene.names)
                 raise UnknownNameError("link or obstacle", name, known_names, where=f"allow of attached '{item.name}'")
 
-        frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
-        mount = frame.placement * item.pose
+        joint, mount = mounted(robot, item)
         thickness = item.margin + (robot.padding.get(item.link, 0.0) if item.padding is None else item.padding)
         bodies += [
             Body(
                 item.name,
-                joint=frame.parentJoint,
+                joint=joint,
                 placement=mount * piece.placement,
                 geometry=piece.geometry,
                 kind="attached",
@@ -141,6 +140,12 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
         ]
 
     return tuple(bodies)
+
+
+def mounted(robot: Robot, item: AttachedObject) -> tuple[int, pin.SE3]:
+    """Return the number of the joint that carries an attached object, and the object's pose in that joint's frame."""
+    frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
+    return frame.parentJoint, frame.placement * item.pose
 
 
 def pieces_of(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:

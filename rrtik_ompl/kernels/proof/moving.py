@@ -19,7 +19,6 @@ from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, block_count, convex_solids, placed_bodies
-from rrtik_ompl.model.robot import Chain
 
 NO_LIMIT = 1 << 62
 _BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)
@@ -122,14 +121,10 @@ class MovedSolids:
 
     Args:
         packed: The table.
-        chain: The tree of joints; needed only for bodies that joints carry, as is ``strokes``.
-        strokes: The largest values of sliding joints [m], shape (joints,).
     """
 
-    def __init__(self, packed: ProofPairs, chain: Chain | None = None, strokes: Vector | None = None) -> None:
+    def __init__(self, packed: ProofPairs) -> None:
         self._packed = packed
-        self._chain = chain
-        self._strokes = strokes
         table = packed.table
         self._records = table.solids.reshape(-1, layout.SOLID_SIZE)
         self._sizes = table.sizes.reshape(-1, layout.SIZE_COUNT)
@@ -154,8 +149,10 @@ class MovedSolids:
         parts = self._parts(number)
         kinds = [solid_kind(body, solid) for solid in own]
         known = np.minimum(self._records[parts, layout.SOLID_KIND], layout.CLOUD).tolist()
-        if self._left == 0 or kinds != known or (body.joint > 0 and self._chain is None):
+        if self._left == 0 or kinds != known:
             return False
+        if body.joint > 0 and any(len(self._packed.groups[k]) > BLOCK for k in self._groups.get(number, ())):
+            return False  # what is around them would not be what packing makes
         if layout.CLOUD in kinds:
             self._put_cloud(parts[0], body)
         firsts = self._records[parts, layout.FIRST_BLOCK]
@@ -177,9 +174,9 @@ class MovedSolids:
                 self._sizes[place] = self._around([k for member in members for k in self._parts(member)])
         around = [self._packed.firsts[-1] + group for group in self._groups.get(number, ())]
         self._packed.spread_sizes([*range(first, end), *around])
-        if self._chain is not None and self._strokes is not None and body.joint > 0:
+        if body.joint > 0:
             packed = self._packed
-            packed.sweeps = packed.sweeps.with_body(number, reaches_of(self._chain, [body], [own], self._strokes)[0])
+            packed.sweeps = packed.sweeps.with_body(number, reaches_of(packed.chain, [body], [own], packed.strokes)[0])
             packed.table.reaches[:] = packed.sweeps.lanes().ravel()
         return True
 

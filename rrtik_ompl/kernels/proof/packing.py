@@ -83,6 +83,8 @@ class ProofPairs:
         groups: Bodies that are one solid together; these solids come last.
         first_group: Number of the first pair of several bodies, which come last.
         sweeps: What moves the bodies of its pairs.
+        chain: The tree of joints.
+        strokes: The largest values of sliding joints [m], shape (joints,).
         kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
             :meth:`keep`, and what they keep between all bodies for rounding and slack.
     """
@@ -100,6 +102,8 @@ class ProofPairs:
     groups: Sequence[Members]
     first_group: int
     sweeps: Sweeps
+    chain: Chain
+    strokes: Vector
     kept: tuple[float, float] = (float("nan"), ROOM)
 
     def keep(self, clearance: float, slack: float = 0.0) -> None:
@@ -276,6 +280,8 @@ def proof_pairs(
         groups=listed.together,
         first_group=count,
         sweeps=swept,
+        chain=chain,
+        strokes=np.broadcast_to(np.asarray(strokes, dtype=np.float64), joints),
     )
     pairs_of_bodies.spread_sizes()
     return pairs_of_bodies
