@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -18,9 +19,9 @@ from bench.shared.run import Run
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.cameras.pictures import read_picture
-from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
-from rrtik_ompl.sensing.markers.detection import find_markers
-from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, table_of
+from rrtik_ompl.sensing.markers import search
+from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS, aligned_corners, mean_side
+from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, is_turned, marker_cells, spare_bits, table_of
 from rrtik_ompl.sensing.sight import MIN_SIDE_PIXELS, as_gray
 
 SEED = 43_000
@@ -30,13 +31,17 @@ MARKERS = 50  # in a map
 LEAST_PICTURES, LEAST_PHOTOGRAPHS = 1000, 150
 # Those with the same first markers find the less, the more markers they have, as fewer bits are corrected.
 STRICTER = {f"{bits}x{bits}_{size}": f"{bits}x{bits}_50" for bits in (4, 5, 6, 7) for size in (100, 250, 1000)}
+SEARCHED = tuple(name for name in DICTIONARIES if name not in STRICTER)
+CORRECTING = "apriltag_36h11"  # a dictionary whose bits are corrected as far as possible in a thorough search
+USUAL_CORRECTION = 0.6  # OpenCV's share of the bits that could be corrected
 HEADS = ("dictionary", "markers in the map", "squares whose bits are a marker's", "largest likeness", "accepted")
 INTRO = (
     f"Crops of {WIDTH} x {HEIGHT} pixels at random places of photographs without markers, each searched for the first "
-    f"{MARKERS} markers of a dictionary (all, if it has fewer), at the settings of `detect_objects`; none is there, so "
-    "that every search goes to its end. Accepted: likeness and size suffice for the pose of an object. "
-    "Dictionaries of one size have the same first markers, and the one of 50 corrects most bits: what the others "
-    "find, it finds, too."
+    f"{MARKERS} markers of every dictionary (all, if it has fewer) at the settings of `detect_objects`. None is there, "
+    "so every search goes to its end. One search serves all: OpenCV's detector compares each square with several "
+    "dictionaries, with as many corrected bits as for each alone. Accepted: likeness and size suffice for the pose of "
+    "an object. Dictionaries of one size have the same first markers, and the one of 50 corrects most bits: what the "
+    "others find, it finds, too."
 )
 
 
@@ -52,13 +57,34 @@ def crops_of(file: str) -> dict[str, list[float]]:
         x, y = int(rng.integers(width - WIDTH + 1)), int(rng.integers(height - HEIGHT + 1))
         crop = np.ascontiguousarray(gray[y : y + HEIGHT, x : x + WIDTH])
         found["pictures"].append(float(crop.std()))
-        for name in DICTIONARIES:
-            if name not in STRICTER:
-                likenesses = [
-                    marker.likeness if marker.side >= MIN_SIDE_PIXELS else -1.0
-                    for marker in find_markers(crop, name, wanted=range(count_of(name)))
-                ]
-                found.setdefault(name, []).extend(likenesses)
+        with patch.object(search, "_detected", detected_of_all):
+            squares = search.search(crop, CORRECTING)
+        for number, corners in squares:
+            name, number = SEARCHED[number // MARKERS], number % MARKERS
+            fit = aligned_corners(crop, corners, marker_cells(name, number), spoilt=spare_bits(name))
+            large = mean_side(fit.corners) >= MIN_SIDE_PIXELS
+            found.setdefault(name, []).append(fit.likeness if large else -1.0)
+    return found
+
+
+def detected_of_all(gray: search.Gray, _: search.Codes, share: float, **how: bool) -> list[search.Found]:
+    """In place of `search._detected`: of all that are `SEARCHED`, whose numbers count on from each to the next."""
+    if min(gray.shape) < 8:
+        return []
+    tables = [search.Codes(name, tuple(range(count_of(name)))).table() for name in SEARCHED]
+    parameters = search._detector(search.Codes(CORRECTING), share, **how).getDetectorParameters()
+    if how.get("thorough"):
+        for name, table in zip(SEARCHED, tables, strict=True):
+            # Only codes that are far apart are corrected as far as they can be; others as far as elsewhere.
+            table.maxCorrectionBits = spare_bits(name) or int(USUAL_CORRECTION * table.maxCorrectionBits)
+    corners, rows, _, which = cv2.aruco.ArucoDetector(tables, parameters).detectMarkersMultiDict(gray)
+    if rows is None:
+        return []
+    found = []
+    for square, row, place in zip(corners, np.ravel(rows), np.ravel(which), strict=True):
+        turned = 2 if is_turned(SEARCHED[place]) else 0
+        outline = np.roll(square.reshape(4, 2).astype(np.float64), turned, axis=0)
+        found.append(search.Found(int(MARKERS * place + row), outline))
     return found
 
 

@@ -7,7 +7,7 @@ import pytest
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.markers import search as searching
-from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
+from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS, aligned_corners
 from rrtik_ompl.sensing.markers.detection import find_markers
 from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
@@ -64,6 +64,19 @@ def test_a_code_of_few_bits_is_accepted_only_if_every_cell_is_right(family, acce
         (marker,) = find_markers(picture, family, wanted=[3])
         assert (marker.likeness >= MIN_LIKENESS) == fine
         assert (marker.spread is not None) == fine
+
+
+@pytest.mark.parametrize("corners", [
+    [[100, 100], [300, 100], [300, 100.01], [100, 100.01]],
+    [[100, 100], [300, 100], [100, 100], [300, 100]],
+    [[100, 100], [300, 300], [200, 200], [150, 150.001]],
+    [[100, 100], [101, 100], [101, 101], [100, 101]],
+])  # fmt: skip
+def test_what_is_no_square_is_not_aligned(corners):
+    """Neither an error, nor a blur that reaches across thousands of samples."""
+    fit = aligned_corners(texture((640, 480)), np.array(corners, dtype=float), marker_cells(FAMILY, 3))
+    assert fit.likeness < MIN_LIKENESS
+    assert fit.spread is None
 
 
 @pytest.fixture

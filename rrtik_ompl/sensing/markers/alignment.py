@@ -45,6 +45,7 @@ _ROUNDS = 3  # rounds of alignment, each with the blur and tone estimated in the
 _LINEAR_BELOW = 0.35
 # Number of samples along a side that suffices for the search of blur and tone.
 _FEW = 48
+_NARROWEST = 3.0  # [pixels]; of a marker in the picture, with its rim: narrower ones cannot be read
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 1e-6)
 
 
@@ -170,6 +171,10 @@ def cell_errors(model: Pixels, seen: Pixels, count: int) -> Vector:
     return np.asarray(np.abs(seen_means - shown_means) / max(float(contrast), 1e-6), dtype=np.float64)
 
 
+class _TooNarrow(Exception):
+    """An alignment has collapsed to less than a marker can be: its blur would reach across thousands of samples."""
+
+
 class _Fit(NamedTuple):
     """The alignment of an ideal marker with a picture.
 
@@ -216,7 +221,7 @@ def _lay_over(
         fit = _align_with_look(ideal, piece, homography.astype(np.float32), tone, last_look)
         if last_look is not None and fit.likeness < MIN_LIKENESS:  # the look of the previous picture was misleading
             fit = _align_with_look(ideal, piece, homography.astype(np.float32), tone, None)
-    except cv2.error:  # the alignment did not converge
+    except (cv2.error, _TooNarrow):  # the alignment did not converge
         return origin, square, None
 
     return origin, square, fit
@@ -330,18 +335,25 @@ def _like_last_look(look: Look, last_look: Look) -> bool:
 
 
 def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
-    """Return the covariance, at the centre of the ideal marker, of a round spot of one pixel in the picture."""
+    """Return the covariance, at the centre of the ideal marker, of a round spot of one pixel in the picture.
+
+    Raises:
+        _TooNarrow: If the marker would be narrower than `_NARROWEST` in the picture.
+    """
     middle = np.array([0.5 * (shape[1] - 1), 0.5 * (shape[0] - 1), 1.0])
     x, y = homography[:2] @ middle
     bottom = homography[2] @ middle
     slope = (homography[:2, :2] - np.outer([x, y], homography[2, :2]) / bottom) / bottom
 
+    narrow_side = np.linalg.svd(slope, compute_uv=False)[-1] * min(shape) if np.isfinite(slope).all() else 0.0
+    if narrow_side < _NARROWEST:
+        raise _TooNarrow
     inverse_slope = np.linalg.inv(slope)
     return np.asarray(inverse_slope @ inverse_slope.T, dtype=np.float64)
 
 
 def _blurred(picture: Pixels, spread: Matrix) -> Pixels:
-    reach = max(int(np.ceil(3.0 * np.sqrt(spread.diagonal().max()))), 1)
+    reach = int(np.clip(np.ceil(3.0 * np.sqrt(spread.diagonal().max())), 1, max(picture.shape)))
     x = np.arange(-reach, reach + 1.0)
     y = x[:, None]
     (a, b), (_, c) = np.linalg.inv(spread)
