@@ -67,21 +67,22 @@ def crops_of(file: str) -> dict[str, list[float]]:
     return found
 
 
-def detected_of_all(gray: search.Gray, _: search.Codes, share: float, **how: bool) -> list[search.Found]:
+def detected_of_all(gray: search.Gray, codes: search.Codes, share: float, **how: bool) -> list[search.Found]:
     """In place of `search._detected`: of all that are `SEARCHED`, whose numbers count on from each to the next."""
     if min(gray.shape) < 8:
         return []
     tables = [search.Codes(name, tuple(range(count_of(name)))).table() for name in SEARCHED]
-    parameters = search._detector(search.Codes(CORRECTING), share, **how).getDetectorParameters()
+    parameters = search._detector(codes, share, **how).getDetectorParameters()
     if how.get("thorough"):
         for name, table in zip(SEARCHED, tables, strict=True):
             # Only codes that are far apart are corrected as far as they can be; others as far as elsewhere.
             table.maxCorrectionBits = spare_bits(name) or int(USUAL_CORRECTION * table.maxCorrectionBits)
-    corners, rows, _, which = cv2.aruco.ArucoDetector(tables, parameters).detectMarkersMultiDict(gray)
+    squares, rows, _, which = cv2.aruco.ArucoDetector(tables, parameters).detectMarkersMultiDict(gray)
     if rows is None:
         return []
     found = []
-    for square, row, place in zip(corners, np.ravel(rows), np.ravel(which), strict=True):
+    places = [int(each) for each in np.ravel(which)]
+    for square, row, place in zip(squares, np.ravel(rows), places, strict=True):
         turned = 2 if is_turned(SEARCHED[place]) else 0
         outline = np.roll(square.reshape(4, 2).astype(np.float64), turned, axis=0)
         found.append(search.Found(int(MARKERS * place + row), outline))
