@@ -281,6 +281,8 @@ def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tm
         goal, chosen = browser.ask("state.goal"), browser.ask("selected")
         spot = browser.ask(SPOT % "crate")
         browser.drag(spot, spot, 1)  # a click selects it
+        browser.ask(FRAMES)
+        spot = browser.ask(SPOT % "crate")  # beside its handles
         browser.drag(spot, [spot[0] + 10.0, spot[1] - 40.0])
         browser.ask(FRAMES)
         moved = browser.ask("[state.obstacles[0].pose[3], state.obstacles[0].pose[7], state.obstacles[0].pose[11]]")

@@ -110,6 +110,7 @@ function newPath() {
   const player = document.getElementById("player");
   if (player.hidden) {
     player.hidden = false;
+    document.getElementById("player-keys").hidden = false;
     viewer.set_3d_pane_size();
   }
   scrub.max = total;

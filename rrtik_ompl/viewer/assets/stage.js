@@ -195,8 +195,9 @@ function setPosture(group, q) {
 // surface alone and looks like tinted glass, not like a heap of overlapping shells. Each is a little farther away than the one before,
 // so that the arm, or else the first of them, is seen where they coincide.
 const DRAWN_GHOSTS = 8;  // as many of all solutions: more would hide each other
+const LEAST_SHARE = 0.02;  // of its box that a solid fills
 const GHOST_UNITS = 16;  // steps of the depth buffer from each ghost to the next one
-let ghostCount = 0;
+const ghosts = [];
 function tintGlass(glass, color) {
   glass.color.set(color);
   glass.emissive.set(color).multiplyScalar(dark.matches ? 0.7 : 0.3);
@@ -211,17 +212,36 @@ const DRAWN_ONCE = {
 };
 const GLASS = { blending: THREE.CustomBlending, blendSrcAlpha: THREE.OneFactor, blendDstAlpha: THREE.OneMinusSrcAlphaFactor };
 
+/** Whether triangles show their fronts to the outside of a volume, so that nobody sees their backs. */
+function isSolid(geometry) {
+  geometry.computeBoundingBox();
+  const { position } = geometry.attributes;
+  const corners = geometry.index?.array ?? [...Array(position.count).keys()];
+  const centre = geometry.boundingBox.getCenter(new THREE.Vector3());
+  const [a, b, c] = [0, 1, 2].map(() => new THREE.Vector3());
+  let volume = 0;
+  for (let k = 0; k + 2 < corners.length; k += 3) {
+    [a, b, c].forEach((corner, n) => corner.fromBufferAttribute(position, corners[k + n]).sub(centre));
+    volume += a.dot(b.cross(c)) / 6;
+  }
+  const box = geometry.boundingBox.getSize(a);
+  return volume > LEAST_SHARE * box.x * box.y * box.z;
+}
+const solids = new Set();
+if (robot) node("robot").traverse((item) => { if (item.isMesh && isSolid(item.geometry)) solids.add(item.geometry); });
+
 function addGhost(name, color, q) {
   const depth = new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true });
   const glass = tintGlass(new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.55, depthWrite: false, ...GLASS }), color);
   const ghost = new THREE.Group();
-  ghostCount += 1;
+  ghosts.push(ghost);
   [depth, glass].forEach((material, pass) => {
-    Object.assign(material, { side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: GHOST_UNITS * ghostCount });
+    Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: GHOST_UNITS * ghosts.length });
+    const twoSided = Object.assign(material.clone(), { side: THREE.DoubleSide });
     const copy = node("robot").clone(true);
     const tipFrame = copy.getObjectByName("tip frame");
     if (tipFrame) tipFrame.parent.remove(tipFrame);
-    copy.traverse((item) => { if (item.isMesh) Object.assign(item, { material, renderOrder: pass + 1, castShadow: false, ...DRAWN_ONCE }); });
+    copy.traverse((item) => { if (item.isMesh) Object.assign(item, { material: solids.has(item.geometry) ? material : twoSided, renderOrder: pass + 1, castShadow: false, ...DRAWN_ONCE }); });
     setPosture(copy, q);
     ghost.add(copy);
   });
@@ -235,6 +255,25 @@ drawnGhosts.forEach((ghost, n) => {
   ghost.color = ghostColors[n];
   addGhost(ghost.name, ghost.color, ghost.q);
 });
+
+/** Whether two links are at the same place, but for rounding. */
+function coincide(a, b) {
+  return a.position.distanceTo(b.position) < 1e-7 * size && Math.abs(a.quaternion.dot(b.quaternion)) > 1 - 1e-12;
+}
+
+/** Where a ghost's link stands on the arm's own nothing of it is seen: it is not drawn. */
+function hideGhostsBehindArm() {
+  const arm = node("robot");
+  const links = new Map(arm.children.map((link) => [link.name, link]));
+  for (const ghost of ghosts) {
+    for (const copy of ghost.children) {
+      for (const link of copy.children) {
+        const own = links.get(link.name);
+        link.visible = !(arm.visible && own && coincide(own, link));
+      }
+    }
+  }
+}
 
 /** Show the piece of the trail that is being travelled in full colour, the others paler; all of them where none is. */
 function highlightPiece(piece) {
@@ -365,6 +404,7 @@ viewer.set_3d_pane_size = () => {
 viewer.set_3d_pane_size();
 const render = viewer.render.bind(viewer);
 viewer.render = () => {
+  hideGhostsBehindArm();
   renewShadows();
   render();
   placeLabels();
