@@ -55,6 +55,7 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
     ("convert",): ("problem.yaml", "other.yaml"),
     ("markers", "print"): ("sheet.pdf",),
     ("markers", "calibrate"): ("photographs", "--out", "camera.yaml"),
+    ("markers", "map"): ("photographs", "--camera-file", "none.yaml", "--out", "map.yaml"),
     ("markers", "sense"): ("none.png", "--camera-file", "none.yaml", "--map", "none.yaml"),
 }
 NO_NUMBERS = {int: ("x", "", "1.5", "nan", "1e3", "0x10"), float: ("x", "", "nan", "inf", "-inf", "1e999", "1,5")}

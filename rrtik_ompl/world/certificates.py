@@ -74,7 +74,7 @@ def _route(path: Certifiable) -> Route:
     """Return how something moves."""
     if isinstance(path, Route):
         return path
-    if isinstance(path, HasRoute):
+    if isinstance(path, HasRoute) and isinstance(path.route, Route):  # a roadmap's is a method
         return path.route
     waypoints = path.waypoints if isinstance(path, HasWaypoints) else path
     return Route(number_rows(waypoints, "waypoints of a certificate"))

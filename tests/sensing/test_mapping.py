@@ -249,7 +249,7 @@ def test_the_command_writes_a_map_that_is_sensed(tmp_path, capsys, pictures):
     CAMERA.save(camera)
     out = tmp_path / "map.yaml"
 
-    given = ("markers", "map", folder, "--camera-file", camera, "--out", out)
+    given = ("markers", "map", folder, "--camera-file", camera, "--out", out, "--dictionary", "4x4_50")
     code, text, err = rrtik(capsys, *given, "--known", "0-1:151.33")
     assert (code, err) == (0, "")
     assert "0 to 1: 151.3" in text

@@ -8,6 +8,7 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.markers.corner_pose import pose_of_points
 from rrtik_ompl.sensing.markers.detection import SeenMarker
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import relative_pose
@@ -92,3 +93,17 @@ def test_the_relative_pose_of_two_objects_is_as_uncertain_as_it_says():
     assert np.mean(found) == pytest.approx(6.0, rel=0.15)
     with pytest.raises(InputError, match="socket"):
         relative_pose(replace(sights[0], refused="covered"), sights[1])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_points_in_any_plane_of_an_object_give_its_pose(seed):
+    rng = np.random.default_rng(seed)
+    flat = np.column_stack([rng.uniform(-0.1, 0.1, (8, 2)), np.zeros(8)])
+    plane = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.1, 3))
+    points = flat @ plane.rotation.T + plane.translation
+    T = pin.SE3(pin.exp3(rng.normal(0.0, 0.5, 3)), np.array([*rng.uniform(-0.1, 0.1, 2), 1.0]))
+    pixels = CAMERA.project(points @ T.rotation.T + T.translation)
+
+    found = pose_of_points(CAMERA, pixels, points)
+    assert found.error < 1e-6
+    assert pin.log6(found.T_camera_object.actInv(T)).vector == pytest.approx(np.zeros(6), abs=1e-7)

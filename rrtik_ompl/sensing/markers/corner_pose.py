@@ -150,8 +150,8 @@ def pose_of_points(
         moving: Whether the displacements are large beside the error of the pixels, as with a rolling shutter: then the
             points are weighted by the inverse of their covariance, so that the pose does not bend to the motion.
     """
-    guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE) if _in_a_plane(points) else []
-    best, other, _ = _branches(camera, points, pixels, guesses or _guesses(camera, points, pixels)[:1])
+    guesses = _guesses_in_a_plane(camera, points, pixels) or _guesses(camera, points, pixels)[:1]
+    best, other, _ = _branches(camera, points, pixels, guesses)
     error, other_error = (np.inf if T is None else _error(camera, points, pixels, T) for T in (best, other))
     covariances = _pixel_covariance(len(points), sigma, spread), _point_covariance(camera, points, best, shifts)
     if moving:
@@ -162,9 +162,18 @@ def pose_of_points(
     return CornerPose(best, other, error, other_error, covariance, surprise, strain)
 
 
-def _in_a_plane(points: Matrix) -> bool:
-    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(extents[2] < _FLAT * extents[0])
+def _guesses_in_a_plane(camera: Camera, points: Matrix, pixels: Matrix) -> list[pin.SE3]:
+    """Return the closed-form poses of points in a plane, best first; none if the points are in no plane."""
+    middle = points.mean(axis=0)
+    _, extents, axes = np.linalg.svd(points - middle, full_matrices=False)
+    if extents[2] >= _FLAT * extents[0]:
+        return []
+
+    # OpenCV's solution is wrong for points in another plane than z = 0.
+    axes[2] = np.cross(axes[0], axes[1])
+    T_plane_object = pin.SE3(axes, -axes @ middle)
+    on_plane = (points - middle) @ axes.T * [1.0, 1.0, 0.0]
+    return [guess * T_plane_object for guess in _guesses(camera, on_plane, pixels, cv2.SOLVEPNP_IPPE)]
 
 
 def _branches(
