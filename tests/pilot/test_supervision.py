@@ -9,7 +9,7 @@ import pytest
 from rrtik_ompl.pilot.interlock import LATE_SECONDS, Sight
 from rrtik_ompl.pilot.machine import READ_SECONDS
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
-from rrtik_tests.hostile_arm import HostileArm, Pilot
+from rrtik_tests.hostile_arm import HostileArm, Pilot, SteppedPilot
 from rrtik_tests.pilot_session import PROBLEM, ROBOT, refused, session
 
 RATES = np.full(ROBOT.dof, np.radians(10.0))
@@ -61,7 +61,7 @@ def test_an_arm_with_a_fault_is_stopped_within_a_degree_and_half_a_second_and_na
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_latched_until_it_is_reset(fault):
-    with Pilot() as pilot:
+    with SteppedPilot() as pilot:
         pilot.hold(0.5)
         pilot.arm.fault = fault
         state = pilot.go_on(10.0, until=lambda state: state["level"] == "alarm")
@@ -83,7 +83,7 @@ def test_a_fault_is_latched_until_it_is_reset(fault):
 
 
 def test_an_arm_that_does_not_stop_is_named():
-    with Pilot() as pilot:
+    with SteppedPilot() as pilot:
         pilot.hold(0.4)
         pilot.arm.fault = "runaway"
         pilot.go_on(0.1)
@@ -95,7 +95,7 @@ def test_an_arm_that_does_not_stop_is_named():
 
 @pytest.mark.parametrize("delay", [0.0, 0.1, 0.3])
 def test_after_the_release_an_arm_moves_a_degree_at_most_over_any_line(delay):
-    with Pilot(delay=delay) as pilot:
+    with SteppedPilot(delay=delay) as pilot:
         begin = pilot.arm._q.copy()
         state = pilot.hold(0.8 + 2.0 * delay)
         released = pilot.arm._q.copy()
@@ -130,7 +130,7 @@ def test_the_rate_falls_as_the_line_gets_slower():
 
 
 def test_a_hold_that_lapses_is_said_and_needs_a_new_press():
-    with Pilot() as pilot:
+    with SteppedPilot() as pilot:
         pilot.hold(0.4)
         state = pilot.look(0.5)
         assert state["level"] == "alarm"
@@ -141,7 +141,7 @@ def test_a_hold_that_lapses_is_said_and_needs_a_new_press():
 
 
 def test_a_page_that_does_not_say_what_it_shows_or_shows_old_pictures_drives_nothing():
-    with Pilot() as pilot:
+    with SteppedPilot() as pilot:
         before = pilot.arm._q.copy()
         pilot.page.say(name="jog", direction=1.0, press=90)
         assert "reload it" in pilot.look(0.2)["message"]

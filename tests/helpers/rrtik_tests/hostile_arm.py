@@ -1,9 +1,11 @@
 """An arm that does another thing than it is told, and a pilot who holds a joint's key at it through a whole server."""
 
+import queue
 import socket
 import threading
 import time
 from contextlib import ExitStack, closing
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.overlay.virtual_camera import pinhole_camera
-from rrtik_ompl.pilot.run import Loop
+from rrtik_ompl.pilot.run import PERIOD_SECONDS, Loop
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.web.server import PilotServer
 from rrtik_tests.browser import PatientLoop
@@ -184,6 +186,9 @@ class Pilot:
         self._thread.join(10)
         self._stack.close()
 
+    def now(self):
+        return time.monotonic()
+
     def look(self, seconds):
         """Show what comes for a while; returns the last state."""
         end = time.monotonic() + seconds
@@ -207,11 +212,100 @@ class Pilot:
 
     def go_on(self, seconds, until=lambda state: False):
         """Hold it on."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end and not until(self._state):
+        end = self.now() + seconds
+        while self.now() < end and not until(self._state):
             self.say("jog", direction=self._direction, press=self._press)
             self.look(0.04)
         return self._state
 
     def release(self):
         self.say("release")
+
+
+class SteppedLoop(Loop):
+    """A loop whose clock is set by a test."""
+
+    now = 0.0
+
+    @property
+    def time(self):
+        return self.now
+
+
+class Desk:
+    """A server and its only page without sockets: what either says reaches the other after a delay [s]."""
+
+    def __init__(self, delay):
+        self._delay, self._to_server, self._to_page = delay, [], []
+        self.now, self.commands = 0.0, queue.Queue()
+        self.clients = OnePage()
+
+    def heard(self):
+        return {}
+
+    def say(self, **words):
+        """The page says something."""
+        self._to_server.append((self.now + self._delay, words))
+
+    def show_state(self, state, executed):
+        self._to_page.append((self.now + self._delay, state))
+
+    def show_frame(self, kind, taken, jpeg):
+        if kind == "C":
+            self._to_page.append((self.now + self._delay, taken))
+
+    def deliver(self):
+        """Hand what has arrived to the server, and return what has arrived at the page."""
+        while self._to_server and self._to_server[0][0] <= self.now:
+            self.commands.put((1, dict(self._to_server.pop(0)[1])))
+        arrived = []
+        while self._to_page and self._to_page[0][0] <= self.now:
+            arrived.append(self._to_page.pop(0)[1])
+        return arrived
+
+
+class OnePage(list):
+    """The pages of a desk: one, which is the pilot."""
+
+    pilot = SimpleNamespace(number=1)
+
+    def __init__(self):
+        super().__init__([self.pilot])
+
+
+class SteppedPilot(Pilot):
+    """The same session and the same hands, on a clock that only the hands advance: no load of the machine matters."""
+
+    TICK = PERIOD_SECONDS / 4.0
+
+    def __init__(self, delay=0.0):
+        self.arm = HostileArm()
+        self.session = Session(PROBLEM, self.arm, seed=1)
+        self.page = Desk(delay)
+        self._loop = SteppedLoop(Undrawn(self.session, Seeing(), simulated=(self.arm,)), self.page)
+        self._ticks = 0
+        self._state, self._seen, self._picture = {}, None, None
+        self._press, self._direction = 0, 1.0
+        self.look(0.6 + 2.0 * delay)
+
+    def __exit__(self, *_):
+        pass
+
+    def now(self):
+        return self.page.now
+
+    def look(self, seconds):
+        """Advance the clock, with a picture every period and commands executed between two pictures."""
+        for _ in range(max(round(seconds / self.TICK), 1)):
+            self._ticks += 1
+            self.page.now = self._loop.now = self._ticks * self.TICK
+            for each in self.page.deliver():
+                if isinstance(each, dict):
+                    self._state, self._seen = each, each["stamp"]
+                else:
+                    self._picture = each
+            if self._ticks % 4 == 0:
+                self._loop._step()
+            while not self.page.commands.empty():
+                self._loop._execute_one(0.0)
+        return self._state
