@@ -264,13 +264,13 @@ class Desk:
         return arrived
 
 
-class OnePage(list):
+class OnePage:
     """The pages of a desk: one, which is the pilot."""
 
     pilot = SimpleNamespace(number=1)
 
-    def __init__(self):
-        super().__init__([self.pilot])
+    def __len__(self):
+        return 1
 
 
 class SteppedPilot(Pilot):
