@@ -141,7 +141,8 @@ def random_poses(quick: bool) -> list[Row]:
         text = (
             f"{arrived[rule].sum()} of {count}; the others end at {_span(nearest[~arrived[rule]])} times the accuracy"
         )
-        label, reading = f"random poses: {rule}", f"at most {most} {BUDGET}"
+        label = f"random poses: {rule}"
+        reading = f"at most {most} {BUDGET}"
         if rule == SLOW_RULE:
             rows.append(Row(label, PRINTED[rule], text, None, f"{reading}; not only goals at limits are slow"))
         else:

@@ -118,10 +118,13 @@ def singular_families(quick: bool) -> list[Row]:
 
 def beside_singular(quick: bool) -> list[Row]:
     """Poses of postures that are singular but for a little, where the digits of a closed form are lost."""
-    robot, rng, count = rrtik.load_robot("titan4"), np.random.default_rng(6), 20 if quick else 100
+    robot = rrtik.load_robot("titan4")
+    rng = np.random.default_rng(6)
+    count = 20 if quick else 100
     rows = []
     for case in ("wrist", "elbow wrist", "shoulder", "shoulder wrist", "all psi"):
-        worst, found = 0.0, 0
+        worst = 0.0
+        found = 0
         for away in BESIDE:
             for pose in robot.fk_batch(_beside(robot, case, away, count, rng)):
                 answer = rrtik.solve_ik(robot, rrtik.PoseGoal(pin.SE3(pose)), method="closed-form")

@@ -149,7 +149,8 @@ def measured(number: int, count: int) -> Row:
     condition = CONDITIONS[number]
     camera = camera_of(condition)
     marker_map = map_of(condition)
-    squares, errors = [], []
+    squares = []
+    errors = []
     for k in range(count):
         truth, picture = photographed(condition, camera, np.random.default_rng([SEED + 400 + number, k]))
         for sight in detect_objects(picture, camera, marker_map):
@@ -158,7 +159,8 @@ def measured(number: int, count: int) -> Row:
                 errors.append(1e3 * float(np.linalg.norm(off(sight.pose.T_camera_object, truth)[:3])))
 
     within = 100.0 * float(np.mean(np.array(squares) <= INSIDE))
-    median, error = float(np.median(squares)), np.quantile(errors, [0.5, 0.95])
+    median = float(np.median(squares))
+    error = np.quantile(errors, [0.5, 0.95])
     cells = [condition.name, str(count), str(len(squares)), f"{error[0]:.2f}", f"{error[1]:.2f}", f"{median:.1f}",
              f"{within:.1f}"]  # fmt: skip
     return Row(cells, within, median)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.sensing.calibration_fit import stepped
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 Stack = NDArray[np.float64]  # arrays of more than two axes
@@ -81,11 +82,6 @@ class Adjustment(NamedTuple):
         of_targets: Covariance of all targets' seven numbers, followed by those of the intrinsics, shape (t, t); 0 where
             nothing is fitted.
         of_cameras: Covariance of the pose of each camera, shape (n, 6, 6).
-        slopes: Slopes of the whitened residuals of each sight by the camera's pose, shape (2 k, 6), and by all other
-            numbers, shape (2 k, t).
-        residuals: The whitened residuals of each sight, shape (2 k,).
-        free: Which of the other numbers are fitted, shape (t,).
-        prior: Their inverse covariance before anything is seen, shape (t, t).
     """
 
     found: Unknowns
@@ -93,10 +89,6 @@ class Adjustment(NamedTuple):
     errors: Vector
     of_targets: Matrix
     of_cameras: Stack
-    slopes: list[tuple[Matrix, Matrix]]
-    residuals: list[Vector]
-    free: NDArray[np.bool_]
-    prior: Matrix
 
     @property
     def error(self) -> float:
@@ -270,10 +262,6 @@ class _Bundle:
             self.errors(found),
             covariance,
             inverse + follow @ covariance @ follow.transpose(0, 2, 1),
-            slopes,
-            residuals,
-            free,
-            self.prior,
         )
 
     def _seen(self, found: Unknowns) -> tuple[Stack, Stack, Stack]:
@@ -308,7 +296,10 @@ class _Bundle:
         return np.concatenate([targets.ravel(), intrinsics(found.lens) - intrinsics(self.stated)])
 
     def _linearised(self, found: Unknowns) -> tuple[list[tuple[Matrix, Matrix]], list[Vector]]:
-        """Return the slopes of whitened residuals, and the residuals, as of `Adjustment`."""
+        """Return the slopes of each sight's whitened residuals, and the residuals, shape (2 k,).
+
+        Slopes are by the camera's pose, shape (2 k, 6), and by all other numbers, shape (2 k, t).
+        """
         views, on_target, at = self._seen(found)
         in_camera = np.einsum("mji,mj->mi", views, at)
         by_point = found.lens.jacobian(in_camera, np.zeros(3))[:, :3].reshape(-1, 2, 3)
@@ -369,11 +360,6 @@ class _Bundle:
 def intrinsics(camera: Camera) -> Vector:
     """Return fx, fy, cx, cy and the coefficients of the lens, shape (4 + k,)."""
     return np.concatenate([camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]], camera.distortion])
-
-
-def stepped(pose: pin.SE3, step: Vector) -> pin.SE3:
-    """Return a pose moved by a position [m] and a rotation about the axes of the frame in which it is given [rad]."""
-    return pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])
 
 
 def _moved(found: Unknowns, stated: Camera, cameras: Matrix, others: Vector) -> Unknowns | None:

@@ -115,7 +115,7 @@ def refined(views: Sequence[View], camera: Camera, poses: Sequence[pin.SE3], fre
 
         moved = _moved(camera, step, free)
         turned = [
-            _stepped(pose, _solved(_damped(of_pose, damping), right - mixed.T @ step))
+            stepped(pose, _solved(_damped(of_pose, damping), right - mixed.T @ step))
             for pose, (_, mixed, of_pose, _, right) in zip(poses, normals, strict=True)
         ]
         new_cost = np.inf if moved is None else _cost(views, moved, turned, prior)
@@ -234,5 +234,6 @@ def _moved(camera: Camera, step: Vector, free: NDArray[np.bool_]) -> Camera | No
     return Camera(matrix, camera.width, camera.height, numbers[4:], lens=camera.lens)
 
 
-def _stepped(pose: pin.SE3, step: Vector) -> pin.SE3:
+def stepped(pose: pin.SE3, step: Vector) -> pin.SE3:
+    """Return a pose moved by a position [m] and a rotation about the axes of the frame in which it is given [rad]."""
     return pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative, whole_number
-from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
+from rrtik_ompl.base.errors import InputError, UnknownNameError, few, listed, require
 from rrtik_ompl.base.poses import quaternion_xyzw
 from rrtik_ompl.sensing.adjustment import OF_POSE, OF_TARGET, Adjustment, Sight, Unknowns, adjusted, intrinsics, robust
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -203,7 +203,9 @@ def map_markers(
     if reference is None:
         reference = numbers[0]
     if reference not in numbers:
-        raise InputError(f"marker {reference} is seen in no picture, but {_few(numbers)}; choose another reference")
+        raise InputError(
+            f"marker {reference} is seen in no picture, but {few(map(str, numbers), 3)}; choose another reference"
+        )
 
     mounted = {number: MountedMarker(number, side_of.get(number, side), side_sigma=side_sigma) for number in numbers}
     return _Mapper(camera, dictionary, reference, mounted, names).mapped(looks)
@@ -362,7 +364,7 @@ class _Mapper:
             bad = [self.names[look.picture][0] for look in group if id(look) in misfits]
             if len(bad) > 1 and len(bad) > _MOST_MISFITS * len(group):
                 raise InputError(
-                    f"marker {number} is elsewhere in {_few(bad)} than in other pictures: it moved between them, its "
+                    f"marker {number} is elsewhere in {few(bad, 3)} than in other pictures: it moved between them, its "
                     "number is printed twice, or its side is another one; take all pictures with everything at rest"
                 )
 
@@ -474,9 +476,3 @@ def _grouped(items: Sequence[Any], name: Callable[[Any], int]) -> dict[int, list
     for item in items:
         groups[name(item)].append(item)
     return dict(sorted(groups.items()))
-
-
-def _few(names: Sequence[object]) -> str:
-    """Return at most three names, and how many more there are."""
-    told = ", ".join(str(name) for name in names[:3])
-    return told if len(names) <= 3 else f"{told} and {len(names) - 3} more"

@@ -9,7 +9,7 @@ the minimum. The covariance follows from first-order propagation of the errors o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -117,15 +117,8 @@ def pose_of_square(
 
     best_pose, other, valley = _branches(camera, points, pixels, guesses)
     other = valley if other is None else other
-    error = _error(camera, points, pixels, best_pose)
-    other_error = np.inf if other is None else _error(camera, points, pixels, other)
-
     covariances = _pixel_covariance(len(points), sigma, spread), _point_covariance(camera, points, best_pose, shifts)
-    if moving:
-        best_pose = _levenberg(camera, points, pixels, best_pose, covariances[0] + covariances[1])
-        other = None if other is None else _levenberg(camera, points, pixels, other, covariances[0] + covariances[1])
-    covariance, surprise = _covariance(camera, points, pixels, best_pose, covariances, moving)
-    return CornerPose(best_pose, other, error, other_error, covariance, surprise)
+    return _judged(camera, points, pixels, (best_pose, other), covariances, moving)
 
 
 def pose_of_points(
@@ -152,14 +145,37 @@ def pose_of_points(
     """
     guesses = _guesses_in_a_plane(camera, points, pixels) or _guesses(camera, points, pixels)[:1]
     best, other, _ = _branches(camera, points, pixels, guesses)
-    error, other_error = (np.inf if T is None else _error(camera, points, pixels, T) for T in (best, other))
     covariances = _pixel_covariance(len(points), sigma, spread), _point_covariance(camera, points, best, shifts)
+    found = _judged(camera, points, pixels, (best, other), covariances, moving)
+    return replace(found, strain=_strain(camera, points, pixels, found.T_camera_object, covariances))
+
+
+def _judged(
+    camera: Camera,
+    points: Matrix,
+    pixels: Matrix,
+    poses: tuple[pin.SE3, pin.SE3 | None],
+    covariances: tuple[Matrix, Matrix],
+    moving: bool,
+) -> CornerPose:
+    """Return the poses with their errors and covariance.
+
+    Args:
+        camera: See `pose_of_points`.
+        points: See `pose_of_points`.
+        pixels: See `pose_of_points`.
+        poses: The pose with the least error, and the second one.
+        covariances: See `_covariance`.
+        moving: See `pose_of_points`.
+    """
+    error, other_error = (np.inf if T is None else _error(camera, points, pixels, T) for T in poses)
+    best, other = poses
     if moving:
-        best = _levenberg(camera, points, pixels, best, covariances[0] + covariances[1])
-        other = None if other is None else _levenberg(camera, points, pixels, other, covariances[0] + covariances[1])
+        both = covariances[0] + covariances[1]
+        best = _levenberg(camera, points, pixels, best, both)
+        other = None if other is None else _levenberg(camera, points, pixels, other, both)
     covariance, surprise = _covariance(camera, points, pixels, best, covariances, moving)
-    strain = _strain(camera, points, pixels, best, covariances)
-    return CornerPose(best, other, error, other_error, covariance, surprise, strain)
+    return CornerPose(best, other, error, other_error, covariance, surprise)
 
 
 def _guesses_in_a_plane(camera: Camera, points: Matrix, pixels: Matrix) -> list[pin.SE3]:

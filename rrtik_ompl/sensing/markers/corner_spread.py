@@ -67,10 +67,11 @@ def corner_spread(
         (8, 3) [pixels].
     """
     step = max(len(model) // _FEW, 1)
-    columns = _columns(model, square, corners, step)
+    across, down = (_slope(model, *way) for way in ((1, 0), (0, 1)))
+    columns = _columns(model, across, down, square, corners, step)
     values = seen[::step, ::step].ravel().astype(np.float64)
     if camera is not None and not camera.is_pinhole:
-        values += _bent_by_lens(camera, model, square, corners, step)
+        values += _bent_by_lens(camera, across[::step, ::step], down[::step, ::step], square, corners, step)
     shape = columns.shape[:2]
     columns = columns.reshape(len(values), -1)
     # Samples within one pixel have the same error.
@@ -106,17 +107,15 @@ def corner_spread(
     return corners + solution[:8].reshape(4, 2), frozen(own + common @ common.T), frozen(common)
 
 
-def _columns(model: Pixels, square: Matrix, corners: Matrix, step: int) -> Matrix:
+def _columns(model: Pixels, across: Matrix, down: Matrix, square: Matrix, corners: Matrix, step: int) -> Matrix:
     """Return the Jacobian of the grey values of the marker with respect to all fitted numbers, shape (h, w, k).
 
     The columns are eight coordinates of corners, then brightness, contrast, spread of ink, three of blur, four bends,
-    and sharpening. Only one sample in ``step`` along each side is used.
+    and sharpening. Only one sample in ``step`` along each side is used. The model's slopes are ``across`` and ``down``.
     """
     radius = _SHARPENED * float(np.sqrt(_area(square) / _area(corners)))
     detail = (model - cv2.GaussianBlur(model, (0, 0), radius))[::step, ::step]
 
-    across = _slope(model, 1, 0)
-    down = _slope(model, 0, 1)
     blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
 
     across = across[::step, ::step]
@@ -136,16 +135,15 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, step: int) -> Matri
     return np.dstack([_slopes(across, down, (x, y), square, corners), *light_and_bends, detail])
 
 
-def _bent_by_lens(camera: Camera, model: Pixels, square: Matrix, corners: Matrix, step: int) -> Vector:
+def _bent_by_lens(camera: Camera, across: Matrix, down: Matrix, square: Matrix, corners: Matrix, step: int) -> Vector:
     """Return how much brighter the samples would be if the lens kept straight lines straight, shape (h w,)."""
-    across, down = (_slope(model, *way)[::step, ::step].ravel() for way in ((1, 0), (0, 1)))
-    samples = np.stack([each.ravel() for each in _sample_places(*model[::step, ::step].shape, step)], axis=1)
+    samples = np.stack([each.ravel() for each in _sample_places(*across.shape, step)], axis=1)
 
     view, on_plane = camera.seen_by_pinhole(corners)
     to_plane, to_picture = _perspectives(np.stack([square, square]), np.stack([on_plane, corners]))
     pixels = camera.project(np.column_stack([_moved(to_plane, samples), np.ones(len(samples))]) @ view.T)
     shift = _moved(np.linalg.inv(to_picture), pixels) - samples
-    return np.asarray(across * shift[:, 0] + down * shift[:, 1], dtype=np.float64)
+    return np.asarray(across.ravel() * shift[:, 0] + down.ravel() * shift[:, 1], dtype=np.float64)
 
 
 def _moved(homography: Matrix, points: Matrix) -> Matrix:

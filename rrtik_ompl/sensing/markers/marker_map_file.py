@@ -136,18 +136,16 @@ def write_into(
     file: str | os.PathLike[str],
     map_file: str | os.PathLike[str],
     *,
-    name: str = "",
-    markers: Sequence[MountedMarker] = (),
-    T_base_camera: pin.SE3 | None = None,
+    name: str,
+    markers: Sequence[MountedMarker],
 ) -> None:
-    """Write a copy of a marker map with other markers on an object, or with another pose of the camera.
+    """Write a copy of a marker map with other markers on an object.
 
     Args:
         file: The file to write, in the same folder if the map names files of meshes.
         map_file: The map.
         name: Name of the object.
-        markers: Its markers, in its frame; those that it has stay if there are none.
-        T_base_camera: Pose of the camera; as it is if None.
+        markers: Its markers, in its frame.
 
     Raises:
         InputError: If there is no such object, the map cannot be read, or the file cannot be written.
@@ -159,15 +157,12 @@ def write_into(
     if files and file_name(file).resolve().parent != document.path.resolve().parent:
         raise InputError(f"{file}: the map names files beside it; write to the folder {document.path.parent}")
 
-    if T_base_camera is not None:
-        data["camera_pose"] = pose_data(T_base_camera)
-    if markers:
-        names = [each["name"] for each in data["objects"]]
-        if name not in names:
-            raise UnknownNameError("object", name, names, where=str(map_file))
-        changed = dict(data["objects"][names.index(name)])
-        changed["markers"] = [_marker_data(marker) for marker in markers]
-        data["objects"] = [changed if each["name"] == name else each for each in data["objects"]]
+    names = [each["name"] for each in data["objects"]]
+    if name not in names:
+        raise UnknownNameError("object", name, names, where=str(map_file))
+    changed = dict(data["objects"][names.index(name)])
+    changed["markers"] = [_marker_data(marker) for marker in markers]
+    data["objects"] = [changed if each["name"] == name else each for each in data["objects"]]
     write_yaml(file, data)
 
 

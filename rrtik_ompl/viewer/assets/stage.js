@@ -227,14 +227,19 @@ function isSolid(geometry) {
   const box = geometry.boundingBox.getSize(a);
   return volume > LEAST_SHARE * box.x * box.y * box.z;
 }
-const solids = new Set();
-if (robot) node("robot").traverse((item) => { if (item.isMesh && isSolid(item.geometry)) solids.add(item.geometry); });
+let solids = null;  // of the arm; looked for when there is a ghost
+function solidsOf(group) {
+  const found = new Set();
+  group.traverse((item) => { if (item.isMesh && isSolid(item.geometry)) found.add(item.geometry); });
+  return found;
+}
 
 function addGhost(name, color, q) {
   const depth = new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true });
   const glass = tintGlass(new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.55, depthWrite: false, ...GLASS }), color);
   const ghost = new THREE.Group();
   ghosts.push(ghost);
+  solids ??= solidsOf(node("robot"));
   [depth, glass].forEach((material, pass) => {
     Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: GHOST_UNITS * ghosts.length });
     const twoSided = Object.assign(material.clone(), { side: THREE.DoubleSide });
