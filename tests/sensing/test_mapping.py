@@ -9,7 +9,8 @@ from scipy.stats import chi2
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing import map_markers
-from rrtik_ompl.sensing.adjustment import Sight, Unknowns, adjusted, stepped
+from rrtik_ompl.sensing.adjustment import Sight, Unknowns, adjusted
+from rrtik_ompl.sensing.calibration_fit import stepped
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
